@@ -86,8 +86,8 @@ class WindowServices(QObject):
         )
         self.training: TrainingDialog | None = None
         self.teaching: TeachingWindow | None = None
-        self._left: list[Callable[[], bool]] = []
-        """Of teachings of other benches: what waits until all is written."""
+        self._still_writing: list[Callable[[], bool]] = []
+        """Each waits until a teaching that was left has written all."""
         self._taught = ""
         self._unfamiliar_s = 0
         self._was_offered: set[str] = set()
@@ -161,8 +161,8 @@ class WindowServices(QObject):
             self.training.end()
         if self.teaching is not None:
             self.teaching.end()
-            self._left.append(self.teaching.model.wait)
-        for wait in self._left:
+            self._still_writing.append(self.teaching.model.wait)
+        for wait in self._still_writing:
             wait()
 
     # ---- sessions
@@ -272,7 +272,7 @@ class WindowServices(QObject):
                 self.teaching.say(tr("Another bench is in use; this one is being trained: wait for it, or stop it"), is_fault=True)
                 return
             self.teaching.end()
-            self._left.append(self.teaching.model.wait)
+            self._still_writing.append(self.teaching.model.wait)
             self.teaching.deleteLater()
             self.teaching = None
         if self.teaching is None:

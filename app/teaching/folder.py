@@ -65,7 +65,7 @@ _THUMB_WIDTH_PX = 152
 _STATE, _BENCH, _VESSEL, _SET = "teaching.json", "bench", "vessel.png", "set"
 _MASKS = "masks"
 _PLANES = "vessel", "robot", "doubtful", "differs"
-"""Masks of a frame, bits of one picture in ``masks/METHOD``: they need not be made again while bench and method are the same."""
+"""Masks of a frame, bits of one picture in ``masks/VERSION``; made again for another bench or ``teaching.MASKS_VERSION``."""
 _OURS = ("empty", "places", "frames", "corrected", _MASKS)
 
 
@@ -661,7 +661,7 @@ class TeachingFolder:
 
 
 def _masks() -> str:
-    return f"{_MASKS}/{teaching.METHOD}"
+    return f"{_MASKS}/{teaching.MASKS_VERSION}"
 
 
 def _not_written(path: Path, error: OSError) -> BenchError:

@@ -213,7 +213,7 @@ class TeachingModel(QObject):
         """
         if self._is_closed or (self.is_busy and not quiet):
             return
-        if not (self.is_loaded or quiet or then == self._on_loaded):
+        if not (self.is_loaded or quiet or then == self._on_loaded):  # with that, the job itself reads or removes it
             self.load()
             return
         self._count += 1

@@ -29,8 +29,8 @@ from core.messages import message
 from core.perception.segmentation import Probability
 from core.types import Image, Mask, Refusal
 
-METHOD = 1
-"""Version of the masks that ``propose`` makes by registration and difference: raise it with these, and kept ones are made again."""
+MASKS_VERSION = 1
+"""Of what ``propose`` makes. Raise it when that, the registration or the difference changes: kept masks are made again."""
 Segment = Callable[[Image], tuple[Probability, Probability]]
 """Vessel and robot probabilities, float32 (h, w) each, of a picture (h, w, 3)."""
 FEWEST = 8

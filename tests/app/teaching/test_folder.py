@@ -184,7 +184,7 @@ def test_everything_is_there_again_after_the_window_was_closed(work: TeachingFol
     assert again.share == pytest.approx(work.view().share)
 
 
-def test_masks_are_made_again_only_for_another_bench_or_method_or_where_they_are_damaged(
+def test_masks_are_made_again_only_for_another_bench_or_version_or_where_they_are_damaged(
     work: TeachingFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drive(work)
@@ -196,9 +196,9 @@ def test_masks_are_made_again_only_for_another_bench_or_method_or_where_they_are
     for taken, again in zip(before, work.view().frames, strict=True):
         for name in ("vessel", "robot", "doubtful", "differs"):
             assert np.array_equal(getattr(taken.frame, name), getattr(again.frame, name))
-    monkeypatch.setattr(teaching, "METHOD", 2)
+    monkeypatch.setattr(teaching, "MASKS_VERSION", 2)
     work = reopened(work, tmp_path)
-    assert len(made) == 1 + len(before), "made by another method"
+    assert len(made) == 1 + len(before), "made by another version"
     work.add_empty(empties(seed=80))
     assert len(made) == 1 + 2 * len(before)
 
