@@ -197,7 +197,7 @@ class AlertStrip(QWidget):
         now = self._clock()
         for alert in alerts:
             before = self._entries.pop(alert.key, None)
-            times = 1 + alert.repeats + (before.times if before is not None else 0)
+            times = max(1, alert.times + (before.times if before is not None else 0))
             self._entries[alert.key] = ShownAlert(alert, times, now)  # the newest one is the last
             if before is None:
                 self._announce(self._entries[alert.key])

@@ -6,6 +6,7 @@ line comes again only after its cooldown.
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -174,17 +175,19 @@ def alert_of(key: AlertKey, *, simulated: bool) -> AlertSpec:
 
 @dataclass(frozen=True, slots=True)
 class Alert:
-    """A line to show now. ``detail`` is the measured value; ``repeats`` counts how often it was suppressed since the last time."""
+    """A line to show now. ``detail`` is the measured value; ``times``: how often it came since it was last shown; 0: it goes on."""
 
     key: AlertKey
     spec: AlertSpec
     detail: str = ""
-    repeats: int = 0
+    times: int = 1
     sound: str | None = None
 
 
 _MOST_ALERTS = 200
 """Alerts that are kept until the window takes them."""
+_SAME_S = 0.5
+"""A line that is raised again within this time goes on: controls are read, and held keys seen, more often."""
 _NO_ALERT = frozenset({RejectReason.NOT_ARMED, RejectReason.WRONG_SOURCE, RejectReason.NO_COMMAND, RejectReason.OUT_OF_ORDER})
 """Rejections that happen in normal driving."""
 
@@ -200,7 +203,8 @@ class AlertReporter:
         self._lock = threading.Lock()
         self._alerts: list[Alert] = []
         self._shown_s: dict[AlertKey, float] = {}
-        self._suppressed: dict[AlertKey, int] = {}
+        self._raised_s: dict[AlertKey, float] = {}
+        self._came: dict[AlertKey, int] = {}
 
     def take(self) -> tuple[Alert, ...]:
         """The alerts since the last call."""
@@ -228,12 +232,14 @@ class AlertReporter:
                 spec = alert_of(key, simulated=self._simulated)
                 always = changed and spec.priority >= Priority.HOLD
                 # a clock that went back ends the cooldown
-                if not always and key in self._shown_s and 0.0 <= now_s - self._shown_s[key] < spec.cooldown_s:
-                    self._suppressed[key] = self._suppressed.get(key, 0) + 1
+                goes_on = 0.0 <= now_s - self._raised_s.get(key, -math.inf) < _SAME_S
+                self._raised_s[key] = now_s
+                self._came[key] = self._came.get(key, 0) + (not goes_on)
+                if not always and 0.0 <= now_s - self._shown_s.get(key, -math.inf) < spec.cooldown_s:
                     continue
                 is_heard = mode in ARMED_MODES and (mode in DRIVING_MODES or spec.priority is not Priority.HOLD)
                 sound = spec.sound if is_heard or spec.priority is Priority.STOP else None
-                alerts.append(Alert(key, spec, detail, self._suppressed.pop(key, 0), sound))
+                alerts.append(Alert(key, spec, detail, self._came.pop(key), sound))
                 self._shown_s[key] = now_s
             alerts.sort(key=lambda alert: -alert.spec.priority)
             sounding = next((place for place, alert in enumerate(alerts) if alert.sound is not None), None)

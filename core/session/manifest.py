@@ -415,7 +415,7 @@ def events_between(before: DriveView | None, after: DriveView) -> Iterator[Event
 
 def event_of_alert(alert: Alert, time_s: float) -> Event:
     """An alert that was shown."""
-    data = {"key": str(alert.key), "detail": alert.detail, "repeats": alert.repeats}
+    data = {"key": str(alert.key), "detail": alert.detail, "times": alert.times}
     return Event(time_s, EventKind.ALERT, alert.spec.text, data)
 
 

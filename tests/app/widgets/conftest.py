@@ -47,8 +47,8 @@ def strip(picture: QWidget, clock: Clock) -> AlertStrip:
     return AlertStrip(picture, clock)
 
 
-def alert(key: AlertKey, detail: str = "", repeats: int = 0) -> Alert:
-    return Alert(key, ALERTS[key], detail, repeats)
+def alert(key: AlertKey, detail: str = "", times: int = 1) -> Alert:
+    return Alert(key, ALERTS[key], detail, times)
 
 
 def words(key: AlertKey) -> str:

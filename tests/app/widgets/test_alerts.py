@@ -32,7 +32,7 @@ STOPPED = DriveView(0.0, Mode.STOPPED, latched=Fault(Cause.TRACKING, "0.8 mm"))
 
 def test_alerts_say_what_is_the_matter_how_much_how_often_and_what_to_do(strip: AlertStrip) -> None:
     assert strip.isHidden()
-    strip.show_alerts([alert(Cause.WARM, "pull left: 66 °C", repeats=2)])
+    strip.show_alerts([alert(Cause.WARM, "pull left: 66 °C", times=3)])
     name, what_to_do = words(Cause.WARM).split(". ")
     assert strip.texts == [f"{name} (pull left: 66 °C) ×3. {what_to_do}"]
     strip.show_alerts([alert(Cause.WARM, "pull left: 67 °C")])

@@ -1,4 +1,4 @@
-"""One table of texts, and repeats that are suppressed."""
+"""One table of texts, and lines that come again."""
 
 import pytest
 
@@ -45,14 +45,21 @@ def test_urgency_and_sound_follow_from_the_reaction(reaction: Reaction, priority
             assert (ALERTS[cause].priority, ALERTS[cause].sound) == (priority, sound)
 
 
-def test_the_same_line_comes_again_only_after_its_cooldown_and_says_how_often_it_was_suppressed() -> None:
+def test_the_same_line_comes_again_only_after_its_cooldown_and_says_how_often_it_came() -> None:
     reporter = AlertReporter()
-    assert [alert.repeats for alert in _report(reporter, Cause.HEAD_JUMP, at_s=10.0)] == [0]
+    assert [alert.times for alert in _report(reporter, Cause.HEAD_JUMP, at_s=10.0)] == [1]
     for at_s in (10.0, 11.0, 12.99):
         assert _report(reporter, Cause.HEAD_JUMP, at_s=at_s) == ()
     assert [alert.key for alert in _report(reporter, Cause.HEAD_JUMP, Cause.STOP_PRESSED, at_s=12.995)] == [Cause.STOP_PRESSED]
-    assert [alert.repeats for alert in _report(reporter, Cause.HEAD_JUMP, at_s=13.0)] == [4]
-    assert [alert.repeats for alert in _report(reporter, Cause.HEAD_JUMP, at_s=16.0)] == [0]
+    assert [alert.times for alert in _report(reporter, Cause.HEAD_JUMP, at_s=13.0)] == [2]  # 11.0 and 12.99
+    assert [alert.times for alert in _report(reporter, Cause.HEAD_JUMP, at_s=16.0)] == [1]
+
+
+def test_a_line_that_goes_on_is_counted_once() -> None:
+    reporter = AlertReporter()
+    shown = [alert.times for turn in range(60) for alert in _report(reporter, Note.AT_LOW_END, at_s=10.0 + turn / 10)]
+    assert shown == [1, 0, 0]  # again after each cooldown of 2 s: it stays on the screen
+    assert [alert.times for alert in _report(reporter, Note.AT_LOW_END, at_s=18.0)] == [1]
 
 
 @pytest.mark.parametrize(
