@@ -327,7 +327,8 @@ def _differs(one: NDArray[np.floating] | Image, other: NDArray[np.floating] | Im
     apart = cv2.GaussianBlur(np.asarray(one, np.float32) - np.asarray(other, np.float32), (0, 0), 2.0)
     slow = cv2.blur(np.clip(apart, -_DIFFERENT_LEVELS, _DIFFERENT_LEVELS), (81, 81))  # no halo around what differs much
     size = np.abs(apart - slow).max(axis=2)
-    seeds = size > np.maximum(_DIFFERENT_SIGMAS * noise / 7.0, _DIFFERENT_LEVELS)  # a Gaussian of 2 px averages 50 pixels
+    least = max(_DIFFERENT_LEVELS, _DIFFERENT_SIGMAS * float(np.median(size)))  # noise may be coloured, and alike in neighbours
+    seeds = size > np.maximum(_DIFFERENT_SIGMAS * noise / 7.0, least)  # a Gaussian of 2 px averages 50 pixels
     return np.asarray(cv2.dilate(seeds.view(np.uint8), np.ones((9, 9), np.uint8)) > 0)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -28,8 +28,8 @@ _LEAST_HIGH, _LEAST_LOW = 14.0, 6.0
 """Least difference (grey levels of Lab, 0 to 255) of a robot's clearest parts, and of its faintest."""
 _HIGH_SIGMAS, _LOW_SIGMAS = 9.0, 4.0
 """The same in deviations of what the rest of the vessel differs by."""
-_NOISY_LEVELS, _NOISY = 3.0, 6.0
-"""Noise of the camera, and of the difference, above which it is smoothed: the thresholds would exceed a robot's contrast."""
+_NOISY = 4.0
+"""Noise of the difference above which it is smoothed: the thresholds would exceed a robot's contrast."""
 _SMOOTH_PX, _HIGH_SMOOTH_SIGMAS, _LOW_SMOOTH_SIGMAS = 1.0, 4.0, 2.3
 """Standard deviation of that smoothing, and the thresholds then: noise alone has no long tail. In the noisiest `tank` the robot's
 Dice rises from 0 to .85."""
@@ -57,7 +57,8 @@ class Difference:
     0.5 at an edge of the robot. ``doubtful``: bool (h, w), places that count neither as robot nor as background
     when a network is trained. ``unusable``: bool (h, w), where a difference says nothing: around a lamp's reflection, and
     over what goes on outside the drawn vessel, such as a cable or a hand. ``chained``: bool (h, w), short parts of the robot that
-    are near others only, bands or a row of bubbles. ``is_noisy``: it was smoothed, and its edges with it.
+    are near others only, bands or a row of bubbles. ``faint``: bool (h, w), where more differs than in most of the vessel, though
+    perhaps too little for a robot. ``is_noisy``: it was smoothed, and its edges with it.
     """
 
     probability: NDArray[np.float32]
@@ -65,6 +66,7 @@ class Difference:
     doubtful: Mask
     unusable: Mask
     chained: Mask
+    faint: Mask
     is_noisy: bool = False
 
 
@@ -112,16 +114,18 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
     probability, evidence, doubtful = np.zeros(image.shape[:2], np.float32), np.zeros(image.shape[:2], np.float32), ~view.known
     x, y, width, height = cv2.boundingRect(view.reachable.view(np.uint8))
     if not width:
-        return Difference(probability, evidence, doubtful, np.zeros_like(doubtful), np.zeros_like(doubtful))
+        nowhere = np.zeros_like(doubtful)
+        return Difference(probability, evidence, doubtful, nowhere, nowhere, nowhere)
     distance = distance_to_empty(image, view)
     unusable = _glare(image)
     box = np.s_[y : y + height, x : x + width]
     allowed = view.reachable[box] & view.known[box] & ~unusable[box]
     noise, sigmas = _deviation(distance[box], allowed), (_HIGH_SIGMAS, _LOW_SIGMAS)
-    is_noisy = noise > _NOISY and float(np.median(view.noise[box][::4, ::4])) > _NOISY_LEVELS
-    if is_noisy:
+    if is_noisy := noise > _NOISY:
         distance = distance_to_empty(image, view, smooth_px=_SMOOTH_PX)
         noise, sigmas = _deviation(distance[box], allowed), (_HIGH_SMOOTH_SIGMAS, _LOW_SMOOTH_SIGMAS)
+    faint = np.zeros_like(doubtful)
+    faint[box] = _faint(distance[box], allowed)
     high, low = max(_LEAST_HIGH, sigmas[0] * noise), max(_LEAST_LOW, sigmas[1] * noise)
     strong = np.where(allowed, distance[box], np.float32(0.0))
     cut = np.maximum(_EDGE_SHARE * _contrast(strong), np.float32(low))
@@ -133,13 +137,7 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
     parts, hopped = _robot_parts(strong, strong > cut, high)
     mask = _with_ends(parts, strong, cut, high)
     mask = cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_CLOSE, _disc(_CLOSE_PX)) > 0
-    shadow = np.zeros(image.shape[:2], np.bool_)
-    shadow[box] = _shadow_beside(mask, image[box], view.lab[box])
-    mask = (
-        np.asarray(cv2.morphologyEx((mask & ~shadow[box]).view(np.uint8), cv2.MORPH_OPEN, _disc(3)) > 0) if shadow.any() else mask
-    )
     values = np.clip(strong / (2.0 * cut), 0.0, 1.0)
-    values[shadow[box]] = 0.0
     bridge = _bridge(mask, view.gradient[box]) & allowed & ~mask
     mask |= bridge
     values[bridge] = np.maximum(values[bridge], np.float32(_UNSEEN))
@@ -149,20 +147,35 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
     if view.window is None:
         _continue_to_border(probability, view.reachable)
     rim = cv2.dilate((probability >= np.float32(0.5)).view(np.uint8), _disc(_RIM_PX)) > 0
-    doubtful |= (distance > np.where(view.reachable, low, high)) & ~rim & ~shadow | unusable
+    doubtful |= (distance > np.where(view.reachable, low, high)) & ~rim | unusable
     chained = np.zeros_like(doubtful)
     if hopped.any():  # with its bridges
         count, labels, _, _ = _components((probability[box] >= np.float32(0.5)) & ~(parts & ~hopped))
         is_chained = np.bincount(labels[hopped], minlength=count) > 0
         is_chained[0] = False
         chained[box] = is_chained[labels]
-    return Difference(probability, evidence, doubtful, unusable, chained, is_noisy)
+    return Difference(probability, evidence, doubtful, unusable, chained, faint, is_noisy)
 
 
 def _deviation(distance: NDArray[np.float32], allowed: Mask) -> float:
     """What pixels (h, w) where a robot may lie differ by, most of which show none: of a normal distribution, by the median."""
     inside = distance[::2, ::2][allowed[::2, ::2]]
     return 1.4826 * float(np.median(inside)) if inside.size else 0.0
+
+
+def _faint(distance: NDArray[np.float32], allowed: Mask) -> Mask:
+    """Where more differs (h, w) than in most of the vessel."""
+    little = cv2.blur(distance, (3, 3))
+    inside = little[::2, ::2][allowed[::2, ::2]]
+    if not inside.size:
+        return np.zeros(distance.shape, np.bool_)
+    middle = float(np.median(inside))
+    spread = 1.4826 * float(np.median(np.abs(inside - middle)))
+    return np.asarray(allowed & (little > middle + max(_FAINT_LEVELS, _FAINT_SIGMAS * spread)), np.bool_)
+
+
+_FAINT_LEVELS, _FAINT_SIGMAS = 2.0, 3.0
+"""By how much, in grey levels and in deviations."""
 
 
 def _foreign(differs: Mask, reachable: Mask) -> Mask:
@@ -273,35 +286,83 @@ _END_BESIDE = 0.15
 """Most of the surroundings of an end that is body: beside the body, where its shadow lies, it is more."""
 
 
-def _shadow_beside(mask: Mask, image: Image, empty: Image) -> Mask:
-    """What of the robot's `mask` (h, w) is the shadow that it casts along all of its length in a lamp's light.
+def beside_network(difference: Difference, network: Probability, image: Image, view: BenchView) -> Difference:
+    """The `difference` of an `image` (h, w, 3), corrected by what the `network` (h, w) sees.
 
-    In a shadow the bench is seen darker, in its own colours. A robot that may itself be that dark is left as it is: nothing but
-    rims would be left of it.
-
-    Parameters
-    ----------
-    empty : the bench, (h, w, 3) in Lab of 8 bits.
+    Without the robot's shadow, and with the parts of the robot that the network sees and that differ little.
     """
-    shadow = np.zeros(mask.shape, np.bool_)
-    if not mask.any():
-        return shadow
+    return _with_faint(_without_shadow(difference, network, image, view), network, view)
+
+
+def _with_faint(difference: Difference, network: Probability, view: BenchView) -> Difference:
+    """The same with what the `network` (h, w) sees apart from the robot, where most of it differs a little."""
+    seen = (network >= np.float32(0.5)) & view.reachable & view.known & ~difference.unusable
+    differing, all_seen = (cv2.blur(one.astype(np.float32), (_FAINT_PX, _FAINT_PX)) for one in (seen & difference.faint, seen))
+    robot = seen & (differing > np.float32(_FAINT_SHARE) * all_seen)
+    found = cv2.dilate((difference.probability >= np.float32(0.5)).view(np.uint8), _square(_APART_PX))
+    apart = cv2.morphologyEx((robot & (found == 0)).view(np.uint8), cv2.MORPH_OPEN, _square(2))
+    if not apart.any():
+        return difference
+    robot &= cv2.dilate(apart, _square(_APART_PX + 2)) > 0
+    probability, evidence = (
+        np.where(robot, np.maximum(of_it, _FAINT), of_it) for of_it in (difference.probability, difference.evidence)
+    )
+    return replace(difference, probability=probability, evidence=evidence)
+
+
+_FAINT_PX, _FAINT_SHARE = 21, 0.6
+"""Side of the square in which this share of what the network sees must differ."""
+_APART_PX = 9
+"""Side of the square around what differs in which the network adds nothing: its outline may be too wide."""
+_FAINT = np.float32(0.55)
+"""Probability and evidence of what differs little."""
+
+
+def _without_shadow(difference: Difference, network: Probability, image: Image, view: BenchView) -> Difference:
+    """The `difference` with the outline of the `network` (h, w) where a lamp's shadow of the robot lies along one side of it.
+
+    In a shadow the bench is seen darker, in its own colours, and the network sees no robot. What it overlooks of a dark robot does
+    not lie on one side of what it sees.
+    """
+    mask = difference.probability >= np.float32(0.5)
+    unseen, least = mask & (network < np.float32(0.5)), _SHADOW_LEAST * np.count_nonzero(mask)
+    if np.count_nonzero(unseen) <= least:
+        return difference
     x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
-    box = np.s_[y : y + height, x : x + width]
-    robot = mask[box]
-    seen, there = (cv2.medianBlur(np.ascontiguousarray(lab), 5).astype(np.float32) for lab in (lab_of(image[box]), empty[box]))
+    rim = _SHADOW_NEAR_PX // 2
+    box = np.s_[max(0, y - rim) : y + height + rim, max(0, x - rim) : x + width + rim]
+    unseen, around = unseen[box], cv2.dilate(mask[box].view(np.uint8), _square(_SHADOW_NEAR_PX)) > 0
+    robot = (network[box] >= np.float32(0.5)) & view.reachable[box] & around
+    if not robot.any():
+        return difference
+    seen, there = (cv2.medianBlur(np.ascontiguousarray(lab), 3).astype(np.float32) for lab in (lab_of(image[box]), view.lab[box]))
     share = (seen[..., 0] + np.float32(_LAB_BLACK)) / (there[..., 0] + np.float32(_LAB_BLACK))
-    colours = seen[..., 1:] - 128.0 - share[..., None] * (there[..., 1:] - 128.0)
-    darker = robot & (share > _SHADOW_SHARE[0]) & (share < _SHADOW_SHARE[1]) & (np.square(colours).sum(axis=2) < _SHADOW_COLOR**2)
-    area, across = np.count_nonzero(robot), _width_px(robot)
-    if np.count_nonzero(darker) < _SHADOW_LEAST * area:
-        return shadow
-    wide = cv2.morphologyEx(darker.view(np.uint8), cv2.MORPH_OPEN, _disc(max(3, 2 * round(_SHADOW_RIM * across) + 1))) > 0
-    rest = cv2.morphologyEx((robot & ~wide).view(np.uint8), cv2.MORPH_OPEN, _disc(3))
-    beside = cv2.dilate(rest, _square(2 * round(across / 2.0) + 1)) > 0
-    if np.count_nonzero(wide) > _SHADOW_LEAST * area and np.count_nonzero(robot & beside) > _SHADOW_BESIDE * area:
-        shadow[box] = wide
-    return shadow
+    colors = seen[..., 1:] - 128.0 - share[..., None] * (there[..., 1:] - 128.0)
+    in_its_colors = np.square(colors).sum(axis=2) < np.float32(_SHADOW_COLOR**2)
+    darker = unseen & (share > _SHADOW_SHARE[0]) & (share < _SHADOW_SHARE[1]) & in_its_colors
+    count, labels, stats, _ = _components(cv2.morphologyEx(darker.view(np.uint8), cv2.MORPH_OPEN, _square(2)))
+    # of the robot about three rows lie within the square's reach
+    touches, across = np.bincount(cv2.dilate(labels, _square(9))[robot], minlength=count) / 3.0, _width_px(robot)
+    is_long = (touches > _SHADOW_LENGTH * across) & (stats[:, cv2.CC_STAT_AREA] >= _LEAST_AREA_PX // 2)
+    is_long[0] = False
+    shadow = is_long[labels]
+    if np.count_nonzero(shadow) <= least or _one_sidedness(darker, robot) < _SHADOW_SIDE:
+        return difference
+    beside = (cv2.dilate(shadow.view(np.uint8), _disc(2 * round(across) + 1)) > 0) & view.reachable[box]
+    probability, evidence, doubtful = difference.probability.copy(), difference.evidence.copy(), difference.doubtful.copy()
+    for values in (probability, evidence):
+        values[box][beside] = network[box][beside]
+    doubtful[box] &= ~shadow
+    return replace(difference, probability=probability, evidence=evidence, doubtful=doubtful)
+
+
+def _one_sidedness(beside: Mask, strand: Mask) -> float:
+    """How much alike the directions are from a `strand` to what lies `beside` it, (h, w) both: 1, all the same in the picture."""
+    _, nearest = cv2.distanceTransformWithLabels((~strand).view(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    places = np.zeros((int(nearest.max()) + 1, 2))
+    places[nearest[strand]] = np.argwhere(strand)
+    away = np.argwhere(beside) - places[nearest[beside]]
+    return float(np.linalg.norm(away.mean(axis=0)) / max(float(np.linalg.norm(away, axis=1).mean()), 1e-6))
 
 
 def _bridge(mask: Mask, gradient: NDArray[np.float32]) -> Mask:
@@ -379,14 +440,15 @@ def _width_px(mask: Mask) -> float:
 
 _LAB_BLACK = 16.0 * 255.0 / 100.0
 """L* + 16, a* and b* are proportional to the cube root of the light (CIE 1976)."""
-_SHADOW_SHARE = 0.55, 0.97
+_SHADOW_SHARE = 0.4, 0.97
 """Of that root, in a robot's shadow: darker is no shadow, lighter is no difference."""
-_SHADOW_COLOR = 5.0
+_SHADOW_COLOR = 10.0
 """Greatest distance of a shadow's colour from the bench's, in levels of Lab."""
-_SHADOW_RIM = 0.1
-"""Half of a rim's width, in widths of robot and shadow: a robot's blurred rim has the bench's colour, too."""
-_SHADOW_LEAST, _SHADOW_BESIDE = 0.3, 0.9
-"""Least share of a shadow in what differs, and of what differs that lies beside the rest."""
+_SHADOW_LEAST, _SHADOW_LENGTH, _SHADOW_NEAR_PX = 0.1, 2.0, 11
+"""Least share of a shadow in what differs, and how far it lies along the robot, in widths of that; the side of the square around
+what differs in which the network's robot counts: a bright robot may differ less than its shadow."""
+_SHADOW_SIDE = 0.7
+"""Least one-sidedness: 0.74 and more in nine of ten frames with a shadow, of four benches of the twin."""
 
 
 def _contrast(strong: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from core.bench.bench import BESIDE_PX, Bench, reachable, read_bench, write_bench
-from core.bench.difference import combined, disagreement, distance_to_empty, robot_by_difference, without_rim
+from core.bench.difference import beside_network, combined, disagreement, distance_to_empty, robot_by_difference, without_rim
 from core.bench.registration import lab_of, register
 from core.config.section import first_problem
 from core.devices import UserError
@@ -29,7 +29,7 @@ from core.messages import message
 from core.perception.segmentation import Probability
 from core.types import Image, Mask, Refusal
 
-MASKS_VERSION = 1
+MASKS_VERSION = 2
 """Of what ``propose`` makes. Raise it when that, the registration or the difference changes: kept masks are made again."""
 Segment = Callable[[Image], tuple[Probability, Probability]]
 """Vessel and robot probabilities, float32 (h, w) each, of a picture (h, w, 3)."""
@@ -62,7 +62,7 @@ _CELL_PX, _KNOWN_SHARE = 40, 0.5
 """Side of a cell in which structure is compared, and the share of it that must be known."""
 _STRONG_SHARE, _LEAST_STRUCTURE = 0.9, 0.009
 """In a cell the strongest tenth of the pixels counts, where its structure is such a share of the brightness."""
-_NOISE_SHARE = 0.5
+_NOISE_SHARE = 1.5
 """And where it exceeds this share of the noise in brightness: the noise that is left in an empty picture is no structure."""
 _HIDDEN, _MOST_HIDDEN = 0.4, 0.12
 """A cell with less than this share of the focus is hidden; share of the cells: at most 0.06 in 80 frames of four benches with
@@ -254,6 +254,8 @@ def propose(picture: TeachingPicture, bench: Bench, segment: Segment | None = No
     robot, doubtful = difference.probability >= np.float32(0.5), difference.doubtful
     if segment is not None:
         network = segment(picture.image)[1]
+        difference = beside_network(difference, network, picture.image, view)
+        doubtful = difference.doubtful
         both = combined(network, difference, view) >= np.float32(0.5)
         core = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
         both = without_rim(network, difference, both & view.known & ~difference.unusable)

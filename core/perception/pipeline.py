@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.bench.bench import Bench, bench_stamp, check_size, reachable, read_bench
-from core.bench.difference import combined, robot_by_difference
+from core.bench.difference import beside_network, combined, robot_by_difference
 from core.bench.registration import BenchView, register, window_of
 from core.config.models import PathConfig, PerceptionConfig
 from core.perception import compiled, quality, robot_path, segmentation, skeleton
@@ -373,7 +373,8 @@ class Pipeline:
         """The robot's probability (h, w) of the network and of the difference to the empty bench."""
         if view.vessel is None:  # where it was not drawn, the robot lies in the vessel that the network sees
             view = replace(view, reachable=reachable(vessel >= self._config.segmentation.vessel_threshold))
-        return combined(robot, robot_by_difference(image, view), view, is_taught=self._stream.is_taught)
+        difference = beside_network(robot_by_difference(image, view), robot, image, view)
+        return combined(robot, difference, view, is_taught=self._stream.is_taught)
 
     def _trace(self, run: _Run, masks: Masks) -> _Structures | Refusal:
         """Skeletons and vessel graph of masks; those of a drawn vessel are known."""

@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 
 from core.bench.bench import Bench, BenchError, bench_from_pictures
-from core.bench.difference import Difference, check_without_robot, combined, disagreement, robot_by_difference, without_rim
+from core.bench.difference import (
+    Difference,
+    beside_network,
+    check_without_robot,
+    combined,
+    disagreement,
+    robot_by_difference,
+    without_rim,
+)
 from core.bench.registration import BenchView, register
 from core.types import Image, Mask
 from tests.core.bench.drawn_bench import SIZE, board, noisy, tube, with_line
@@ -292,19 +300,68 @@ def with_shadow(image: Image, shadow: Mask) -> Image:
     return np.asarray(image * shade[..., None], np.uint8)
 
 
-@pytest.mark.parametrize("color", [(30, 30, 30), (250, 250, 250), (200, 40, 40)])
+def with_network(image: Image, bench: Bench, network: np.ndarray) -> Difference:
+    view = register(image, bench)
+    assert isinstance(view, BenchView), view
+    return beside_network(robot_by_difference(image, view), network, image, view)
+
+
+@pytest.mark.parametrize("color", [(30, 30, 30), (110, 110, 110), (250, 250, 250), (200, 40, 40)])
 def test_the_shadow_that_a_robot_casts_beside_itself_is_no_robot(bench: Bench, color: tuple[int, int, int]) -> None:
     (x, y), (to_x, to_y) = ROBOT
     shadow = line((x, y + 7), (to_x, to_y + 7))
     image = noisy(with_line(with_shadow(board(), shadow), *ROBOT, color), 2.0, 3)
-    difference = found(image, bench)
+    difference = with_network(image, bench, seen_by_network(line(*ROBOT)))
     assert dice(difference.probability >= 0.5, line(*ROBOT)) > 0.9
     assert (difference.doubtful & shadow).sum() < 0.2 * shadow.sum(), "that it is background is learnt"
 
 
-def test_a_robot_as_dark_as_a_shadow_stays_whole(bench: Bench) -> None:
+def test_beside_its_shadow_a_robot_as_bright_as_the_bench_is_where_the_network_sees_it(bench: Bench) -> None:
+    (x, y), (to_x, to_y) = ROBOT
+    image = noisy(with_shadow(board(), line((x, y + 7), (to_x, to_y + 7))), 2.0, 3)
+    robot = line(*ROBOT)
+    assert dice(found(image, bench).probability >= 0.5, robot) < 0.3
+    assert dice(with_network(image, bench, seen_by_network(robot)).probability >= 0.5, robot) > 0.85
+
+
+@pytest.mark.parametrize(
+    "seen",
+    [
+        line((0, 122), (200, 130), 3),
+        line((0, 122), (200, 130)) & (np.arange(SIZE[0]) % 40 < 20),
+        line((0, 119), (100, 123), 3) | line((100, 129), (200, 133), 3),
+        line((280, 20), (300, 20)),
+    ],
+    ids=["its middle", "pieces", "one side and then the other", "something else"],
+)
+def test_a_robot_as_dark_as_a_shadow_stays_whole_where_the_network_overlooks_some_of_it(bench: Bench, seen: Mask) -> None:
     image = noisy(with_shadow(board(), line(*ROBOT)), 2.0, 3)
-    assert dice(found(image, bench).probability >= 0.5, line(*ROBOT)) > 0.9
+    assert dice(with_network(image, bench, seen_by_network(seen)).probability >= 0.5, line(*ROBOT)) > 0.9
+
+
+@pytest.mark.parametrize("where", [ROBOT, ((280, 20), (300, 20)), ((210, 131), (300, 135))], ids=["robot", "outside", "nothing"])
+def test_what_the_network_sees_and_differs_a_little_is_robot(bench: Bench, where: tuple[tuple[int, int], tuple[int, int]]) -> None:
+    faint, tip = tuple(int(level) - 9 for level in board()[130, 206]), line((160, 128), (200, 130))
+    image = noisy(with_line(with_line(board(), *ROBOT, faint), (160, 128), (200, 130), (250, 250, 250)), 1.5, 3)
+    assert dice(found(image, bench).probability >= 0.5, tip) > 0.8, "alone it is too faint beside so clear a tip"
+    robot = with_network(image, bench, seen_by_network(line(*where))).probability >= 0.5
+    assert dice(robot, line(*ROBOT) if where == ROBOT else tip) > 0.8
+
+
+def smooth_noise(image: Image, sigma: float, seed: int) -> Image:
+    """With the noise of a camera that smooths it, so that neighbours have the same."""
+    noise = cv2.GaussianBlur(np.random.default_rng(seed).normal(0, 1, image.shape).astype(np.float32), (0, 0), 1.5)
+    return np.asarray(np.clip(image + noise * (sigma / noise.std()), 0, 255), np.uint8)
+
+
+@pytest.mark.parametrize("pictures", [1, 2, 4])
+def test_in_smooth_noise_one_picture_of_the_empty_bench_is_enough(pictures: int) -> None:
+    bench = bench_from_pictures([smooth_noise(board(), 5.0, seed) for seed in range(pictures)], tube(), "b", 320)
+    assert bench.known.mean() > 0.98, "noise is no change"
+    image = smooth_noise(with_line(board(), *ROBOT, (90, 90, 90)), 5.0, 9)
+    view, difference = register(image, bench), with_network(image, bench, seen_by_network(line(*ROBOT)))
+    assert isinstance(view, BenchView)
+    assert dice(combined(seen_by_network(line(*ROBOT)), difference, view) >= 0.5, line(*ROBOT)) > 0.9
 
 
 def test_a_taught_network_denies_a_shadow_and_not_a_robot_that_it_overlooks(bench: Bench) -> None:
