@@ -310,7 +310,7 @@ def _with_faint(difference: Difference, network: Probability, view: BenchView) -
     return replace(difference, probability=probability, evidence=evidence)
 
 
-_FAINT_PX, _FAINT_SHARE = 21, 0.6
+_FAINT_PX, _FAINT_SHARE = 21, 0.8
 """Side of the square in which this share of what the network sees must differ."""
 _APART_PX = 9
 """Side of the square around what differs in which the network adds nothing: its outline may be too wide."""
@@ -325,7 +325,7 @@ def _without_shadow(difference: Difference, network: Probability, image: Image, 
     not lie on one side of what it sees.
     """
     mask = difference.probability >= np.float32(0.5)
-    unseen, least = mask & (network < np.float32(0.5)), _SHADOW_LEAST * np.count_nonzero(mask)
+    unseen, least = mask & (network < np.float32(_SHADOW_UNSEEN)), _SHADOW_LEAST * np.count_nonzero(mask)
     if np.count_nonzero(unseen) <= least:
         return difference
     x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
@@ -339,14 +339,16 @@ def _without_shadow(difference: Difference, network: Probability, image: Image, 
     share = (seen[..., 0] + np.float32(_LAB_BLACK)) / (there[..., 0] + np.float32(_LAB_BLACK))
     colors = seen[..., 1:] - 128.0 - share[..., None] * (there[..., 1:] - 128.0)
     in_its_colors = np.square(colors).sum(axis=2) < np.float32(_SHADOW_COLOR**2)
-    darker = unseen & (share > _SHADOW_SHARE[0]) & (share < _SHADOW_SHARE[1]) & in_its_colors
+    across = _width_px(robot)
+    apart, nearest = cv2.distanceTransformWithLabels((~robot).view(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    darker = unseen & (share > _SHADOW_SHARE[0]) & (share < _SHADOW_SHARE[1]) & in_its_colors & (apart < _SHADOW_REACH * across)
     count, labels, stats, _ = _components(cv2.morphologyEx(darker.view(np.uint8), cv2.MORPH_OPEN, _square(2)))
     # of the robot about three rows lie within the square's reach
-    touches, across = np.bincount(cv2.dilate(labels, _square(9))[robot], minlength=count) / 3.0, _width_px(robot)
+    touches = np.bincount(cv2.dilate(labels, _square(9))[robot], minlength=count) / 3.0
     is_long = (touches > _SHADOW_LENGTH * across) & (stats[:, cv2.CC_STAT_AREA] >= _LEAST_AREA_PX // 2)
     is_long[0] = False
     shadow = is_long[labels]
-    if np.count_nonzero(shadow) <= least or _one_sidedness(darker, robot) < _SHADOW_SIDE:
+    if np.count_nonzero(shadow) <= least or _one_sidedness(darker, robot, nearest) < _SHADOW_SIDE:
         return difference
     beside = (cv2.dilate(shadow.view(np.uint8), _disc(2 * round(across) + 1)) > 0) & view.reachable[box]
     probability, evidence, doubtful = difference.probability.copy(), difference.evidence.copy(), difference.doubtful.copy()
@@ -356,9 +358,11 @@ def _without_shadow(difference: Difference, network: Probability, image: Image, 
     return replace(difference, probability=probability, evidence=evidence, doubtful=doubtful)
 
 
-def _one_sidedness(beside: Mask, strand: Mask) -> float:
-    """How much alike the directions are from a `strand` to what lies `beside` it, (h, w) both: 1, all the same in the picture."""
-    _, nearest = cv2.distanceTransformWithLabels((~strand).view(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+def _one_sidedness(beside: Mask, strand: Mask, nearest: NDArray[np.int32]) -> float:
+    """How much alike the directions are from a `strand` to what lies `beside` it, (h, w) both: 1, all the same in the picture.
+
+    `nearest`: labels of the strand's nearest pixel.
+    """
     places = np.zeros((int(nearest.max()) + 1, 2))
     places[nearest[strand]] = np.argwhere(strand)
     away = np.argwhere(beside) - places[nearest[beside]]
@@ -447,6 +451,8 @@ _SHADOW_COLOR = 10.0
 _SHADOW_LEAST, _SHADOW_LENGTH, _SHADOW_NEAR_PX = 0.1, 2.0, 11
 """Least share of a shadow in what differs, and how far it lies along the robot, in widths of that; the side of the square around
 what differs in which the network's robot counts: a bright robot may differ less than its shadow."""
+_SHADOW_UNSEEN, _SHADOW_REACH = 0.25, 2.5
+"""The network's probability of a robot there is less; how far from what it sees a shadow reaches, in widths of that."""
 _SHADOW_SIDE = 0.7
 """Least one-sidedness: 0.74 and more in nine of ten frames with a shadow, of four benches of the twin."""
 
