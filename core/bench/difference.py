@@ -348,7 +348,7 @@ def _without_shadow(difference: Difference, network: Probability, image: Image, 
     is_long = (touches > _SHADOW_LENGTH * across) & (stats[:, cv2.CC_STAT_AREA] >= _LEAST_AREA_PX // 2)
     is_long[0] = False
     shadow = is_long[labels]
-    if np.count_nonzero(shadow) <= least or _one_sidedness(darker, robot, nearest) < _SHADOW_SIDE:
+    if np.count_nonzero(shadow) <= least or _one_sidedness(darker, robot, np.asarray(nearest, np.int32)) < _SHADOW_SIDE:
         return difference
     beside = (cv2.dilate(shadow.view(np.uint8), _disc(2 * round(across) + 1)) > 0) & view.reachable[box]
     probability, evidence, doubtful = difference.probability.copy(), difference.evidence.copy(), difference.doubtful.copy()
