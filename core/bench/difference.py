@@ -28,8 +28,10 @@ _LEAST_HIGH, _LEAST_LOW = 14.0, 6.0
 """Least difference (grey levels of Lab, 0 to 255) of a robot's clearest parts, and of its faintest."""
 _HIGH_SIGMAS, _LOW_SIGMAS = 9.0, 4.0
 """The same in deviations of what the rest of the vessel differs by."""
-_NOISY = 4.0
+_UNSMOOTH = 4.0
 """Noise of the difference above which it is smoothed: the thresholds would exceed a robot's contrast."""
+_NOISY, _NOISY_LEVELS = 6.0, 3.0
+"""Noise of the difference, and of the camera, above which the smoothed outlines are too rough, and the network's count."""
 _SMOOTH_PX, _HIGH_SMOOTH_SIGMAS, _LOW_SMOOTH_SIGMAS = 1.0, 4.0, 2.3
 """Standard deviation of that smoothing, and the thresholds then: noise alone has no long tail. In the noisiest `tank` the robot's
 Dice rises from 0 to .85."""
@@ -57,8 +59,8 @@ class Difference:
     0.5 at an edge of the robot. ``doubtful``: bool (h, w), places that count neither as robot nor as background
     when a network is trained. ``unusable``: bool (h, w), where a difference says nothing: around a lamp's reflection, and
     over what goes on outside the drawn vessel, such as a cable or a hand. ``chained``: bool (h, w), short parts of the robot that
-    are near others only, bands or a row of bubbles. ``faint``: bool (h, w), where more differs than in most of the vessel, though
-    perhaps too little for a robot. ``is_noisy``: it was smoothed, and its edges with it.
+    are near others only, bands or a row of bubbles. ``excess``: float32 (h, w), by how many deviations more differs than in most of
+    the vessel: perhaps too little for a robot. ``is_noisy``: its outlines are rough.
     """
 
     probability: NDArray[np.float32]
@@ -66,7 +68,7 @@ class Difference:
     doubtful: Mask
     unusable: Mask
     chained: Mask
-    faint: Mask
+    excess: NDArray[np.float32]
     is_noisy: bool = False
 
 
@@ -114,18 +116,18 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
     probability, evidence, doubtful = np.zeros(image.shape[:2], np.float32), np.zeros(image.shape[:2], np.float32), ~view.known
     x, y, width, height = cv2.boundingRect(view.reachable.view(np.uint8))
     if not width:
-        nowhere = np.zeros_like(doubtful)
-        return Difference(probability, evidence, doubtful, nowhere, nowhere, nowhere)
+        return Difference(probability, evidence, doubtful, np.zeros_like(doubtful), np.zeros_like(doubtful), evidence)
     distance = distance_to_empty(image, view)
     unusable = _glare(image)
     box = np.s_[y : y + height, x : x + width]
     allowed = view.reachable[box] & view.known[box] & ~unusable[box]
     noise, sigmas = _deviation(distance[box], allowed), (_HIGH_SIGMAS, _LOW_SIGMAS)
-    if is_noisy := noise > _NOISY:
+    is_noisy = noise > _NOISY and float(np.median(view.noise[box][::4, ::4])) > _NOISY_LEVELS
+    if noise > _UNSMOOTH:
         distance = distance_to_empty(image, view, smooth_px=_SMOOTH_PX)
         noise, sigmas = _deviation(distance[box], allowed), (_HIGH_SMOOTH_SIGMAS, _LOW_SMOOTH_SIGMAS)
-    faint = np.zeros_like(doubtful)
-    faint[box] = _faint(distance[box], allowed)
+    excess = np.zeros_like(evidence)
+    excess[box] = _excess(distance[box], allowed)
     high, low = max(_LEAST_HIGH, sigmas[0] * noise), max(_LEAST_LOW, sigmas[1] * noise)
     strong = np.where(allowed, distance[box], np.float32(0.0))
     cut = np.maximum(_EDGE_SHARE * _contrast(strong), np.float32(low))
@@ -154,7 +156,7 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
         is_chained = np.bincount(labels[hopped], minlength=count) > 0
         is_chained[0] = False
         chained[box] = is_chained[labels]
-    return Difference(probability, evidence, doubtful, unusable, chained, faint, is_noisy)
+    return Difference(probability, evidence, doubtful, unusable, chained, excess, is_noisy)
 
 
 def _deviation(distance: NDArray[np.float32], allowed: Mask) -> float:
@@ -163,19 +165,19 @@ def _deviation(distance: NDArray[np.float32], allowed: Mask) -> float:
     return 1.4826 * float(np.median(inside)) if inside.size else 0.0
 
 
-def _faint(distance: NDArray[np.float32], allowed: Mask) -> Mask:
-    """Where more differs (h, w) than in most of the vessel."""
+def _excess(distance: NDArray[np.float32], allowed: Mask) -> NDArray[np.float32]:
+    """By how many deviations a pixel (h, w) differs more than most of the vessel, from its surroundings of 3 px."""
     little = cv2.blur(distance, (3, 3))
     inside = little[::2, ::2][allowed[::2, ::2]]
     if not inside.size:
-        return np.zeros(distance.shape, np.bool_)
+        return np.zeros_like(distance)
     middle = float(np.median(inside))
-    spread = 1.4826 * float(np.median(np.abs(inside - middle)))
-    return np.asarray(allowed & (little > middle + max(_FAINT_LEVELS, _FAINT_SIGMAS * spread)), np.bool_)
+    spread = max(1.4826 * float(np.median(np.abs(inside - middle))), _LEAST_SPREAD)
+    return np.asarray(np.where(allowed, np.minimum((little - middle) / spread, _MOST_EXCESS), 0.0), np.float32)
 
 
-_FAINT_LEVELS, _FAINT_SIGMAS = 2.0, 3.0
-"""By how much, in grey levels and in deviations."""
+_LEAST_SPREAD, _MOST_EXCESS = 1.0, 8.0
+"""Least deviation, in grey levels, and the excess that counts at most."""
 
 
 def _foreign(differs: Mask, reachable: Mask) -> Mask:
@@ -295,34 +297,51 @@ def beside_network(difference: Difference, network: Probability, image: Image, v
 
 
 def _with_faint(difference: Difference, network: Probability, view: BenchView) -> Difference:
-    """The same with what the `network` (h, w) sees apart from the robot, where most of it differs a little."""
+    """The same with what the `network` (h, w) sees of the robot beyond what was found, where it differs a little.
+
+    It goes on from what was found, or else is long. It is doubtful where not most of it differs clearly: a clip over the robot
+    shows nothing of it, and its edges differ.
+    """
+    found = difference.probability >= np.float32(0.5)
     seen = (network >= np.float32(0.5)) & view.reachable & view.known & ~difference.unusable
-    differing, all_seen = (cv2.blur(one.astype(np.float32), (_FAINT_PX, _FAINT_PX)) for one in (seen & difference.faint, seen))
-    robot = seen & (differing > np.float32(_FAINT_SHARE) * all_seen)
-    found = cv2.dilate((difference.probability >= np.float32(0.5)).view(np.uint8), _square(_APART_PX))
-    apart = cv2.morphologyEx((robot & (found == 0)).view(np.uint8), cv2.MORPH_OPEN, _square(2))
-    if not apart.any():
+    apart = (seen & (cv2.dilate(found.view(np.uint8), _square(_APART_PX)) == 0)).view(np.uint8)
+    if not cv2.morphologyEx(apart, cv2.MORPH_OPEN, _square(2)).any():
         return difference
+    side = (_FAINT_PX, _FAINT_PX)
+    all_seen = cv2.blur(seen.astype(np.float32), side)
+    excess = cv2.blur(np.where(seen, difference.excess, np.float32(0.0)), side)
+    robot = seen & (excess > np.float32(_FAINT_EXCESS) * all_seen)
+    apart = cv2.morphologyEx((robot & (apart > 0)).view(np.uint8), cv2.MORPH_OPEN, _square(2))
     robot &= cv2.dilate(apart, _square(_APART_PX + 2)) > 0
+    count, labels, _, _ = _components(cv2.dilate((robot | found).view(np.uint8), _square(_GAP_PX)))
+    areas = np.bincount(labels[robot], minlength=count)
+    goes_on = np.bincount(labels[found], minlength=count) > 0 if found.any() else areas >= _LEAST_FAINT_PX
+    robot &= goes_on[labels]
+    clear = cv2.blur((seen & (difference.excess > np.float32(_CLEAR_EXCESS))).astype(np.float32), side)
+    doubtful = difference.doubtful | (robot & (clear < np.float32(_CLEAR_PART) * all_seen))
     probability, evidence = (
         np.where(robot, np.maximum(of_it, _FAINT), of_it) for of_it in (difference.probability, difference.evidence)
     )
-    return replace(difference, probability=probability, evidence=evidence)
+    return replace(difference, probability=probability, evidence=evidence, doubtful=doubtful)
 
 
-_FAINT_PX, _FAINT_SHARE = 21, 0.8
-"""Side of the square in which this share of what the network sees must differ."""
+_FAINT_PX, _FAINT_EXCESS = 21, 2.0
+"""Side of the square in which what the network sees must have this excess on average."""
+_CLEAR_EXCESS, _CLEAR_PART = 3.0, 0.8
+"""Excess of a pixel that differs by itself, and the share of such pixels where a network may learn that this is a robot."""
 _APART_PX = 9
 """Side of the square around what differs in which the network adds nothing: its outline may be too wide."""
+_LEAST_FAINT_PX = 240
+"""Area of a robot that differs a little all along: 60 px of length, 4 px wide."""
 _FAINT = np.float32(0.55)
 """Probability and evidence of what differs little."""
 
 
 def _without_shadow(difference: Difference, network: Probability, image: Image, view: BenchView) -> Difference:
-    """The `difference` with the outline of the `network` (h, w) where a lamp's shadow of the robot lies along one side of it.
+    """The `difference` without a lamp's shadow of the robot along one side of what the `network` (h, w) sees of it.
 
-    In a shadow the bench is seen darker, in its own colours, and the network sees no robot. What it overlooks of a dark robot does
-    not lie on one side of what it sees.
+    In a shadow the bench is seen darker, in its own colours, but otherwise than the robot, and the network sees no robot. Beside it
+    the network's robot counts, too: a bright robot may differ less than its shadow.
     """
     mask = difference.probability >= np.float32(0.5)
     unseen, least = mask & (network < np.float32(_SHADOW_UNSEEN)), _SHADOW_LEAST * np.count_nonzero(mask)
@@ -333,7 +352,8 @@ def _without_shadow(difference: Difference, network: Probability, image: Image, 
     box = np.s_[max(0, y - rim) : y + height + rim, max(0, x - rim) : x + width + rim]
     unseen, around = unseen[box], cv2.dilate(mask[box].view(np.uint8), _square(_SHADOW_NEAR_PX)) > 0
     robot = (network[box] >= np.float32(0.5)) & view.reachable[box] & around
-    if not robot.any():
+    clear = robot & (mask[box] | (difference.excess[box] > np.float32(_CLEAR_EXCESS)))
+    if not clear.any() or clear.sum() < _SHADOW_CLEAR * robot.sum():
         return difference
     seen, there = (cv2.medianBlur(np.ascontiguousarray(lab), 3).astype(np.float32) for lab in (lab_of(image[box]), view.lab[box]))
     share = (seen[..., 0] + np.float32(_LAB_BLACK)) / (there[..., 0] + np.float32(_LAB_BLACK))
@@ -344,16 +364,24 @@ def _without_shadow(difference: Difference, network: Probability, image: Image, 
     darker = unseen & (share > _SHADOW_SHARE[0]) & (share < _SHADOW_SHARE[1]) & in_its_colors & (apart < _SHADOW_REACH * across)
     count, labels, stats, _ = _components(cv2.morphologyEx(darker.view(np.uint8), cv2.MORPH_OPEN, _square(2)))
     # of the robot about three rows lie within the square's reach
-    touches = np.bincount(cv2.dilate(labels, _square(9))[robot], minlength=count) / 3.0
-    is_long = (touches > _SHADOW_LENGTH * across) & (stats[:, cv2.CC_STAT_AREA] >= _LEAST_AREA_PX // 2)
+    contact_px = np.bincount(cv2.dilate(labels, _square(9))[clear], minlength=count) / 3.0
+    is_long = (contact_px > _SHADOW_CONTACT * across) & (stats[:, cv2.CC_STAT_AREA] >= _LEAST_AREA_PX // 2)
     is_long[0] = False
     shadow = is_long[labels]
     if np.count_nonzero(shadow) <= least or _one_sidedness(darker, robot, np.asarray(nearest, np.int32)) < _SHADOW_SIDE:
         return difference
+    levels = seen - there
+    of_shadow, of_robot = (np.median(levels[part], axis=0) for part in (shadow, clear))
+    if float(np.linalg.norm(of_shadow - of_robot)) < _SHADOW_CONTRAST:
+        return difference
     beside = (cv2.dilate(shadow.view(np.uint8), _disc(2 * round(across) + 1)) > 0) & view.reachable[box]
+    is_like_it = (np.square(levels - of_shadow) - np.square(levels - of_robot)).sum(axis=2) < 0
+    shadow |= (cv2.dilate(shadow.view(np.uint8), _square(5)) > 0) & (network[box] < 0.5) & is_like_it
     probability, evidence, doubtful = difference.probability.copy(), difference.evidence.copy(), difference.doubtful.copy()
     for values in (probability, evidence):
-        values[box][beside] = network[box][beside]
+        part = values[box]
+        part[beside] = np.maximum(part, network[box])[beside]
+        part[shadow] = network[box][shadow]
     doubtful[box] &= ~shadow
     return replace(difference, probability=probability, evidence=evidence, doubtful=doubtful)
 
@@ -448,9 +476,12 @@ _SHADOW_SHARE = 0.4, 0.97
 """Of that root, in a robot's shadow: darker is no shadow, lighter is no difference."""
 _SHADOW_COLOR = 10.0
 """Greatest distance of a shadow's colour from the bench's, in levels of Lab."""
-_SHADOW_LEAST, _SHADOW_LENGTH, _SHADOW_NEAR_PX = 0.1, 2.0, 11
-"""Least share of a shadow in what differs, and how far it lies along the robot, in widths of that; the side of the square around
-what differs in which the network's robot counts: a bright robot may differ less than its shadow."""
+_SHADOW_LEAST, _SHADOW_CONTACT, _SHADOW_NEAR_PX = 0.1, 2.0, 11
+"""Least share of a shadow in what differs, and how far it touches the robot, in widths of that; the side of the square around what
+differs in which the network's robot counts."""
+_SHADOW_CLEAR, _SHADOW_CONTRAST = 0.6, 10.0
+"""Share of what the network sees that must differ: else it is something beside the robot. Least distance, in levels of Lab, of what
+shadow and robot differ by from the bench: else it is the robot's other side."""
 _SHADOW_UNSEEN, _SHADOW_REACH = 0.25, 2.5
 """The network's probability of a robot there is less; how far from what it sees a shadow reaches, in widths of that."""
 _SHADOW_SIDE = 0.7

@@ -231,10 +231,10 @@ class AlertReporter:
             for key, detail in raised:
                 spec = alert_of(key, simulated=self._simulated)
                 always = changed and spec.priority >= Priority.HOLD
-                # a clock that went back ends the cooldown
                 goes_on = 0.0 <= now_s - self._raised_s.get(key, -math.inf) < _SAME_S
                 self._raised_s[key] = now_s
                 self._came[key] = self._came.get(key, 0) + (not goes_on)
+                # a clock that went back ends the cooldown
                 if not always and 0.0 <= now_s - self._shown_s.get(key, -math.inf) < spec.cooldown_s:
                     continue
                 is_heard = mode in ARMED_MODES and (mode in DRIVING_MODES or spec.priority is not Priority.HOLD)

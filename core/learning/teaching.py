@@ -62,8 +62,8 @@ _CELL_PX, _KNOWN_SHARE = 40, 0.5
 """Side of a cell in which structure is compared, and the share of it that must be known."""
 _STRONG_SHARE, _LEAST_STRUCTURE = 0.9, 0.009
 """In a cell the strongest tenth of the pixels counts, where its structure is such a share of the brightness."""
-_NOISE_SHARE = 1.5
-"""And where it exceeds this share of the noise in brightness: the noise that is left in an empty picture is no structure."""
+_NOISE_TIMES = 1.5
+"""And where it exceeds the noise in brightness so many times: the noise that is left in an empty picture is no structure."""
 _HIDDEN, _MOST_HIDDEN = 0.4, 0.12
 """A cell with less than this share of the focus is hidden; share of the cells: at most 0.06 in 80 frames of four benches with
 robots, glare, shadows and cables, above 0.2 with a hand in them."""
@@ -291,7 +291,7 @@ def structure_of(image: Image, empty: Image, known: Mask, noise: NDArray[np.floa
     levels, does not count), and the share of cells that are hidden: they show less than ``_HIDDEN`` of it.
     """
     seen, there = _fine_structure(image), _fine_structure(empty)
-    floor = np.float32(_NOISE_SHARE) * noise / (cv2.cvtColor(empty, cv2.COLOR_RGB2GRAY).astype(np.float32) + np.float32(_SHADE))
+    floor = np.float32(_NOISE_TIMES) * noise / (cv2.cvtColor(empty, cv2.COLOR_RGB2GRAY).astype(np.float32) + np.float32(_SHADE))
     shares = []
     for y in range(0, image.shape[0] - _CELL_PX + 1, _CELL_PX):
         for x in range(0, image.shape[1] - _CELL_PX + 1, _CELL_PX):
