@@ -299,7 +299,7 @@ def beside_network(difference: Difference, network: Probability, image: Image, v
 def _with_faint(difference: Difference, network: Probability, view: BenchView) -> Difference:
     """The same with what the `network` (h, w) sees of the robot beyond what was found, where it differs a little.
 
-    It goes on from what was found, or else is long. It is doubtful where not most of it differs clearly: a clip over the robot
+    It goes on from what was found, or else is long, and shows no edge of the bench, which a robot would hide. It is doubtful where not most of it differs clearly: a clip over the robot
     shows nothing of it, and its edges differ.
     """
     found = difference.probability >= np.float32(0.5)
@@ -317,6 +317,11 @@ def _with_faint(difference: Difference, network: Probability, view: BenchView) -
     areas = np.bincount(labels[robot], minlength=count)
     goes_on = np.bincount(labels[found], minlength=count) > 0 if found.any() else areas >= _LEAST_FAINT_PX
     robot &= goes_on[labels]
+    count, labels, _, _ = _components(robot & ~found)
+    for label in range(1, count):
+        part = labels == label
+        if float(np.quantile(view.gradient[part], 0.9)) > _BRIDGE_EDGE:
+            robot &= ~part
     clear = cv2.blur((seen & (difference.excess > np.float32(_CLEAR_EXCESS))).astype(np.float32), side)
     doubtful = difference.doubtful | (robot & (clear < np.float32(_CLEAR_PART) * all_seen))
     probability, evidence = (
@@ -479,7 +484,7 @@ _SHADOW_COLOR = 10.0
 _SHADOW_LEAST, _SHADOW_CONTACT, _SHADOW_NEAR_PX = 0.1, 2.0, 11
 """Least share of a shadow in what differs, and how far it touches the robot, in widths of that; the side of the square around what
 differs in which the network's robot counts."""
-_SHADOW_CLEAR, _SHADOW_CONTRAST = 0.6, 10.0
+_SHADOW_CLEAR, _SHADOW_CONTRAST = 0.6, 4.0
 """Share of what the network sees that must differ: else it is something beside the robot. Least distance, in levels of Lab, of what
 shadow and robot differ by from the bench: else it is the robot's other side."""
 _SHADOW_UNSEEN, _SHADOW_REACH = 0.25, 2.5
