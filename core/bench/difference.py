@@ -299,8 +299,8 @@ def beside_network(difference: Difference, network: Probability, image: Image, v
 def _with_faint(difference: Difference, network: Probability, view: BenchView) -> Difference:
     """The same with what the `network` (h, w) sees of the robot beyond what was found, where it differs a little.
 
-    It goes on from what was found, or else is long, and shows no edge of the bench, which a robot would hide. It is doubtful where not most of it differs clearly: a clip over the robot
-    shows nothing of it, and its edges differ.
+    It goes on from what was found, or else is long, and no edge of the bench shows in it, which a robot would hide. It is doubtful
+    where not most of it differs clearly.
     """
     found = difference.probability >= np.float32(0.5)
     seen = (network >= np.float32(0.5)) & view.reachable & view.known & ~difference.unusable

@@ -132,6 +132,26 @@ def test_a_frame_that_is_not_plausible_is_rejected_by_name(
     assert len(checked[-1].reason.splitlines()) == 1
 
 
+def _plain(robot: Mask | None, seed: int) -> Image:
+    """A bench without structure but its lumen and a few labels, in the noise of a camera that smooths it."""
+    picture = np.where(toy_vessel()[:, :, None], np.float32(160), np.float32(110)) * np.ones(3, np.float32)
+    for x, y in ((30, 30), (130, 40), (60, 200), (160, 200), (240, 215), (250, 120)):
+        cv2.rectangle(picture, (x, y), (x + 24, y + 14), (210, 210, 190), 3)
+    if robot is not None:
+        picture[robot] = (30, 40, 60)
+    noise = np.random.default_rng(seed).normal(0, 1, picture.shape).astype(np.float32)
+    noise = cv2.GaussianBlur(noise, (0, 0), 0.8)
+    return np.asarray(np.clip(cv2.GaussianBlur(picture, (0, 0), 1.0) + noise * (3.0 / noise.std()), 0, 255), np.uint8)
+
+
+def test_noise_left_in_the_empty_pictures_is_no_structure_that_a_frame_could_hide() -> None:
+    bench = _bench(_plain(None, 900), _plain(None, 901))
+    for index in range(4):
+        image = _plain(toy_robot(0, 0.5 + 0.1 * index), index)
+        assert propose(TeachingPicture("frame", "frame", image), bench).reason == ""
+        assert propose(TeachingPicture("hand", "hand", _hand(image)), bench).reason
+
+
 def _cut(frame: TeachingFrame, *columns: slice) -> TeachingFrame:
     robot = frame.robot.copy()
     for cut in columns:
