@@ -28,7 +28,7 @@ _LEAST_HIGH, _LEAST_LOW = 14.0, 6.0
 """Least difference (grey levels of Lab, 0 to 255) of a robot's clearest parts, and of its faintest."""
 _HIGH_SIGMAS, _LOW_SIGMAS = 9.0, 4.0
 """The same in deviations of what the rest of the vessel differs by."""
-_UNSMOOTH = 4.0
+_SMOOTHED_FROM = 4.0
 """Noise of the difference above which it is smoothed: the thresholds would exceed a robot's contrast."""
 _NOISY, _NOISY_LEVELS = 6.0, 3.0
 """Noise of the difference, and of the camera, above which the smoothed outlines are too rough, and the network's count."""
@@ -123,7 +123,7 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
     allowed = view.reachable[box] & view.known[box] & ~unusable[box]
     noise, sigmas = _deviation(distance[box], allowed), (_HIGH_SIGMAS, _LOW_SIGMAS)
     is_noisy = noise > _NOISY and float(np.median(view.noise[box][::4, ::4])) > _NOISY_LEVELS
-    if noise > _UNSMOOTH:
+    if noise > _SMOOTHED_FROM:
         distance = distance_to_empty(image, view, smooth_px=_SMOOTH_PX)
         noise, sigmas = _deviation(distance[box], allowed), (_HIGH_SMOOTH_SIGMAS, _LOW_SMOOTH_SIGMAS)
     excess = np.zeros_like(evidence)
@@ -317,11 +317,13 @@ def _with_faint(difference: Difference, network: Probability, view: BenchView) -
     areas = np.bincount(labels[robot], minlength=count)
     goes_on = np.bincount(labels[found], minlength=count) > 0 if found.any() else areas >= _LEAST_FAINT_PX
     robot &= goes_on[labels]
-    count, labels, _, _ = _components(robot & ~found)
+    count, labels, stats, _ = _components(robot & ~found)
     for label in range(1, count):
-        part = labels == label
-        if float(np.quantile(view.gradient[part], 0.9)) > _BRIDGE_EDGE:
-            robot &= ~part
+        x, y, width, height = stats[label, :4].tolist()
+        box = np.s_[y : y + height, x : x + width]
+        part = labels[box] == label
+        if float(np.quantile(view.gradient[box][part], 0.9)) > _BRIDGE_EDGE:
+            robot[box] &= ~part
     clear = cv2.blur((seen & (difference.excess > np.float32(_CLEAR_EXCESS))).astype(np.float32), side)
     doubtful = difference.doubtful | (robot & (clear < np.float32(_CLEAR_PART) * all_seen))
     probability, evidence = (
