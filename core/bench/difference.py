@@ -384,6 +384,9 @@ def _without_shadow(difference: Difference, network: Probability, image: Image, 
     beside = (cv2.dilate(shadow.view(np.uint8), _disc(2 * round(across) + 1)) > 0) & view.reachable[box]
     is_like_it = (np.square(levels - of_shadow) - np.square(levels - of_robot)).sum(axis=2) < 0
     shadow |= (cv2.dilate(shadow.view(np.uint8), _square(5)) > 0) & (network[box] < 0.5) & is_like_it
+    rest = (mask[box] | robot) & ~shadow
+    thin = rest & ~robot & (cv2.morphologyEx(rest.view(np.uint8), cv2.MORPH_OPEN, _disc(3)) == 0)
+    shadow |= thin & (cv2.dilate(shadow.view(np.uint8), _square(5)) > 0)  # the shadow's blurred rim
     probability, evidence, doubtful = difference.probability.copy(), difference.evidence.copy(), difference.doubtful.copy()
     for values in (probability, evidence):
         part = values[box]
