@@ -190,13 +190,13 @@ def test_masks_are_made_again_only_for_another_bench_or_version_or_where_they_ar
     drive(work)
     before, made, propose = work.view().frames, list[str](), teaching.propose
     monkeypatch.setattr(teaching, "propose", lambda picture, *more: made.append(picture.stem) or propose(picture, *more))
-    (tmp_path / "teaching" / "masks" / "1" / "0001.png").write_bytes(b"no picture")
+    (tmp_path / "teaching" / "masks" / str(teaching.MASKS_VERSION) / "0001.png").write_bytes(b"no picture")
     work = reopened(work, tmp_path)
     assert made == ["0001"]
     for taken, again in zip(before, work.view().frames, strict=True):
         for name in ("vessel", "robot", "doubtful", "differs"):
             assert np.array_equal(getattr(taken.frame, name), getattr(again.frame, name))
-    monkeypatch.setattr(teaching, "MASKS_VERSION", 2)
+    monkeypatch.setattr(teaching, "MASKS_VERSION", teaching.MASKS_VERSION + 1)
     work = reopened(work, tmp_path)
     assert len(made) == 1 + len(before), "made by another version"
     work.add_empty(empties(seed=80))
