@@ -56,8 +56,8 @@ LEAST_NOISE = 0.5
 """Grey levels: what rounding to whole levels, and a camera's own denoising, hide."""
 _DIFFERENT_SIGMAS, _DIFFERENT_LEVELS = 6.0, 10.0
 """Smoothed pictures that differ by more than both, noise deviations and grey levels, do not show the same there."""
-_MOST_NOISY_LEVELS = 30.0
-"""Nor can noise explain more: half of a picture may show something else."""
+_MOST_SMOOTH_NOISE = 30.0
+"""Grey levels of what differs that noise explains at most: more than half of a picture may show something else."""
 _LEAST_FRAMES = 3
 _AGREED_SHARE = 0.5
 """Share of the frames that must show the same, for the empty bench to be known at a pixel."""
@@ -329,10 +329,9 @@ def _differs(one: NDArray[np.floating] | Image, other: NDArray[np.floating] | Im
     apart = cv2.GaussianBlur(np.asarray(one, np.float32) - np.asarray(other, np.float32), (0, 0), 2.0)
     slow = cv2.blur(np.clip(apart, -_DIFFERENT_LEVELS, _DIFFERENT_LEVELS), (81, 81))  # no halo around what differs much
     size = np.abs(apart - slow).max(axis=2)
-    noisy = min(_DIFFERENT_SIGMAS * float(np.median(size)), _MOST_NOISY_LEVELS)  # noise may be coloured, and alike in neighbours
-    seeds = size > np.maximum(
-        _DIFFERENT_SIGMAS * noise / 7.0, max(_DIFFERENT_LEVELS, noisy)
-    )  # a Gaussian of 2 px averages 50 pixels
+    # a Gaussian of 2 px averages 50 pixels of white noise; that of a camera may be alike in neighbours, and coloured
+    smooth_noise = min(_DIFFERENT_SIGMAS * float(np.median(size)), _MOST_SMOOTH_NOISE)
+    seeds = size > np.maximum(_DIFFERENT_SIGMAS * noise / 7.0, max(_DIFFERENT_LEVELS, smooth_noise))
     return np.asarray(cv2.dilate(seeds.view(np.uint8), np.ones((9, 9), np.uint8)) > 0)
 
 

@@ -65,7 +65,7 @@ _STRONG_SHARE, _LEAST_STRUCTURE = 0.9, 0.009
 _NOISE_TIMES = 1.5
 """And where it exceeds the noise in brightness so many times: the noise that is left in an empty picture is no structure."""
 _HIDDEN, _MOST_HIDDEN = 0.4, 0.12
-"""A cell with less than this share of the focus is hidden; share of the cells: at most 0.06 in 80 frames of four benches with
+"""A cell with less than this share of the focus is hidden; share of the cells: at most 0.07 in 80 frames of four benches with
 robots, glare, shadows and cables, above 0.2 with a hand in them."""
 _WIDTHS = (0.4, 2.2)
 """Width of a robot against the median of all frames."""

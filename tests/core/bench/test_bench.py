@@ -27,6 +27,15 @@ def test_a_cable_in_one_of_three_pictures_is_left_out() -> None:
     assert np.array_equal(bench.vessel, tube())
 
 
+@pytest.mark.parametrize("share", [0.3, 0.65])
+def test_a_cloth_over_much_of_one_of_two_pictures_is_not_known(share: float) -> None:
+    covered, columns = board().astype(np.float32), int(share * SIZE[0])
+    covered[:, :columns] += 45 * np.sign(np.sin(np.arange(columns) / 9.0))[None, :, None]  # folds: no change of light
+    picture = np.asarray(np.clip(covered, 0, 255), np.uint8)
+    known = bench_from_pictures([noisy(board(), 2.0, 1), noisy(picture, 2.0, 2)], None, "b", 320).known
+    assert known[:, :columns].mean() < 0.6 and known[:, columns + 40 :].mean() > 0.95
+
+
 def test_where_two_pictures_differ_the_bench_is_not_known() -> None:
     bench = bench_from_pictures([noisy(board(), 2.0, 1), with_line(noisy(board(), 2.0, 2), (20, 20), (300, 60))], None, "b", 320)
     assert not bench.known[40, 160]
